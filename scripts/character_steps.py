@@ -25,7 +25,7 @@ from scripts.knees_bench import legs
 from scripts.rigs_bench import measured, middle
 from spark.evaluation.metrics import mean_score
 from spark.training.same_motion import same_motion
-from spark.transfer import analytic, foot_lock, hip_sway, leg_fit, over_floor, refine
+from spark.transfer import analytic, foot_lock, hip_sway, leg_fit, over_floor, own_soles, refine
 from spark.transfer.canonical import CanonicalMotion
 from spark_sim.clips import Clip
 
@@ -59,6 +59,7 @@ NOTHING = np.array([1.0, 0.0, 0.0, 0.0])
 WITHOUT: dict[str, tuple[ModuleType, Callable[..., object]]] = {
     "from_rest_to_rest": (analytic, lambda source, moved: moved),
     "travel_scale": (leg_fit, lambda source, target: target.hip_height / source.hip_height),
+    "on_own_soles": (own_soles, lambda source, moved, *_: moved),
     "_lying": (leg_fit, lambda source: np.zeros(len(source))),
     "_held": (foot_lock, lambda theirs, own, *_: np.zeros_like(own)),
     "_rolled": (foot_lock, lambda *soles: tuple(sole[..., :2].mean(axis=1) for sole in soles[:2])),

@@ -29,7 +29,7 @@ from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_fit import fit_legs
+from spark.transfer.own_soles import fit_body
 from spark.transfer.refine import refined
 
 SWING_SPEED, SWING_HEIGHT, MIN_SWINGS = 0.5, 0.02, 30  # [m/s], [m] of a truth's swinging sole
@@ -39,9 +39,9 @@ WORST = 6  # characters that are named
 METHODS: dict[str, Callable[[CanonicalMotion, Rig], CanonicalMotion]] = {
     "copy": transfer,
     "copy, feet held": lambda s, rig: lock_feet(s, transfer(s, rig)),
-    "legs fitted": lambda s, rig: fit_legs(s, transfer(s, rig)),
-    "legs fitted, feet held": lambda s, rig: lock_feet(s, fit_legs(s, transfer(s, rig))),
-    "`retarget`": lambda s, rig: refined(s, fit_legs(s, transfer(s, rig))),
+    "legs fitted": lambda s, rig: fit_body(s, transfer(s, rig)),
+    "legs fitted, feet held": lambda s, rig: lock_feet(s, fit_body(s, transfer(s, rig))),
+    "`retarget`": lambda s, rig: refined(s, fit_body(s, transfer(s, rig))),
 }
 
 

@@ -24,7 +24,7 @@ from spark.rig.roles import LIMBS, Group
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_fit import fit_legs
+from spark.transfer.own_soles import fit_body
 from spark.transfer.refine import refined
 from spark_sim.clips import Clip
 
@@ -64,7 +64,7 @@ def main(seconds: str, *paths: str) -> None:
     sources = [spark_sim.load(path) for path in paths[:split]]
     methods: dict[str, Callable[[CanonicalMotion, Rig], CanonicalMotion]] = {
         "copy, feet held": lambda s, rig: lock_feet(s, transfer(s, rig)),
-        "`retarget`": lambda s, rig: refined(s, fit_legs(s, transfer(s, rig))),
+        "`retarget`": lambda s, rig: refined(s, fit_body(s, transfer(s, rig))),
     }
     heads = ("median", "95th percentile", "20° more", "all, mean", "stretched")
     print(f"| | {' | '.join(heads)} |\n|{'---|' * (len(heads) + 1)}")

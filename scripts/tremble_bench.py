@@ -23,8 +23,8 @@ from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
-from spark.transfer.leg_fit import fit_legs
 from spark.transfer.noise import without_noise
+from spark.transfer.own_soles import fit_body
 from spark.transfer.refine import refined
 
 FPS, SECONDS = 30.0, 8.0
@@ -58,7 +58,7 @@ def main() -> None:
 def retargeted(source: CanonicalMotion, rig: Rig, *, smooth: bool) -> CanonicalMotion:
     """As `spark_sim.retarget`, without a network."""
     source, noise, _ = without_noise(source) if smooth else (source, None, ())
-    return refined(source, fit_legs(source, transfer(source, rig)), noise)
+    return refined(source, fit_body(source, transfer(source, rig)), noise)
 
 
 def judged(made: Motion, wanted: Motion, rig: Rig, source: Subject) -> list[float]:

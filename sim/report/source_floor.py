@@ -11,7 +11,7 @@ from sim.report.measures import floor_height
 from sim.report.thresholds import PLAUSIBILITY
 from sim.trajectory import Subject
 from spark.resample import values_at
-from spark.rig.standing import on_zero, same_feet
+from spark.rig.standing import STEADY, on_zero, same_feet
 from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.ground import Ground, level_ground
 from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
@@ -19,7 +19,6 @@ from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
 _MAX_FLOOR_OFFSET = 0.1
-_STEADY = 0.011  # hip heights: a centimetre of an adult
 _DECILES = (10, 50, 90)
 
 
@@ -80,7 +79,7 @@ def _under_own_soles(course: Course, source: Course, scaled: float) -> Ground | 
         return None
     low, middle, high = np.percentile(over, _DECILES)
     own = scaled + float(middle)
-    steady = high - low < _STEADY * course.rig.hip_height
+    steady = high - low < STEADY * course.rig.hip_height
     other = abs(middle) > PLAUSIBILITY.scaled(course.rig.hip_height).penetration
     return level_ground(own) if steady and other and on_zero(course.rig, own) else None
 

@@ -27,7 +27,7 @@ from spark.transfer.canonical import (
     canonical_positions,
     to_canonical,
 )
-from spark.transfer.leg_fit import fit_legs
+from spark.transfer.own_soles import fit_body
 from spark.transfer.refine import grounded, refined
 from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
@@ -111,7 +111,7 @@ def as_method(
     target_prior: bool = False,
     legs_fitted: bool = False,
     feet_held: bool = False,
-    legs: LegFitter = fit_legs,
+    legs: LegFitter = fit_body,
 ) -> Method:
     """A retarget method as `evaluate` takes one.
 

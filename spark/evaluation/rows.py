@@ -13,7 +13,7 @@ from spark.training.dataset import Performance
 from spark.training.recorded_pairs import recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
 from spark.transfer.analytic import transfer
-from spark.transfer.leg_fit import fit_legs
+from spark.transfer.own_soles import fit_body
 from spark.transfer.target_prior import RetargetMethod
 
 _Ways = dict[str, dict[str, bool]]
@@ -83,7 +83,7 @@ def _rows(
     name: str,
     method: RetargetMethod,
     ways: _Ways,
-    legs: LegFitter = fit_legs,
+    legs: LegFitter = fit_body,
     whys: Sequence[Why] = (),
     of_legs: Sequence[Why] = (),
     settings: Mapping[str, object] | None = None,

@@ -14,12 +14,13 @@ def filled_in(
 ) -> CanonicalMotion:
     """`source` on the rig of `recording`: joints without a counterpart as the network of
     `checkpoint` (the one that ships, where that is None) fills them in, and as the target moves
-    them in `recording`; the legs fitted. A network that says where every joint is has said all of
-    that. Raises `FileFormatError` where the checkpoint is none."""
+    them in `recording`; the legs fitted, on its own soles. A network that says where every joint is
+    has said all of that. Raises `FileFormatError` where the checkpoint is none."""
     network = _shipped() if checkpoint is None else NetworkRetargeter(read_weights(checkpoint))
     if not network.network.config.residual:
         return network(source, recording.rig)
-    return network.fit_legs(source, with_target_prior(network, source, recording))
+    moved = with_target_prior(network, source, recording)
+    return network.fit_legs(source, moved, recording)
 
 
 @cache

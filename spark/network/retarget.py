@@ -34,7 +34,7 @@ from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
-from spark.transfer.leg_fit import fit_legs
+from spark.transfer.own_soles import fit_body, on_own_soles
 
 _WINDOWS_AT_ONCE = 32  # bounds memory
 
@@ -97,21 +97,28 @@ class NetworkRetargeter:
             hips=start.hips + values_at(blended.hips - start_30fps.hips, at),
         )
 
-    def fit_legs(self, source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+    def fit_legs(
+        self,
+        source: CanonicalMotion,
+        moved: CanonicalMotion,
+        recording: CanonicalMotion | None = None,
+    ) -> CanonicalMotion:
         """`moved`, the transfer of `source`, with its legs fitted: by the two bodies' proportions,
+        on its own soles (`spark.transfer.own_soles`: `recording` is a motion of the target's own),
         and where the network learned from recorded pairs, and met bodies like these two, as
         these have it (`spark.network.recorded`)."""
         if self.recorded is None:
-            return fit_legs(source, moved)
+            return fit_body(source, moved, recording)
         bodies = tokens_of(source.rig), tokens_of(moved.rig)
         known = self.recorded.known
         share = known.nearness(bodies[0]) * known.nearness(bodies[1])
         moved = replace(moved, notes=(*moved.notes, known.told(*bodies)))
         if not share:
-            return fit_legs(source, moved)
+            return fit_body(source, moved, recording)
         told = self.recorded.told
         doubt = told.doubt(*bodies)
-        return as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
+        fitted = as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
+        return on_own_soles(source, fitted, recording, 1.0 - share)
 
     def _blend_windows(
         self,

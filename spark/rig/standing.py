@@ -13,7 +13,9 @@ from spark.rig.rig import Rig
 # [hip heights] On 37 characters of an animation library, all of which stand on z = 0, it is 0 to
 # 0.034, in the mean 0.009. By a centimetre of an adult more feet hover in recordings, and toes dip
 # by half of that.
-_THICKEST, _HOVER, _DIP = 0.035, 0.011, 0.0055
+THICKEST, USUAL = 0.035, 0.01
+_HOVER, _DIP = 0.011, 0.0055
+STEADY = 0.011  # [hip heights] that soles' heights may spread by: a centimetre of an adult
 # [hip heights] by which the points of two feet that are the same may differ. Of such feet soles are
 # as thick; of feet that differ by 0.003 to 0.01 they differ by 0.008 in the median, and as much of
 # all others.
@@ -23,7 +25,7 @@ _SAME = 0.003
 def on_zero(rig: Rig, soles_z: float) -> bool:
     """Whether a body whose soles are so high [m] may stand on z = 0, in shoes or without. Nothing
     stands lower than it does barefoot."""
-    return -_DIP <= soles_z / rig.hip_height <= _THICKEST + _HOVER
+    return -_DIP <= soles_z / rig.hip_height <= THICKEST + _HOVER
 
 
 def same_feet(one: Rig, other: Rig) -> bool:
