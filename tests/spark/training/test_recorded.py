@@ -30,12 +30,12 @@ from spark.training.recorded_likeness import fit_likeness, surest
 from spark.training.recorded_pairs import RecordedPairs, recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import canonical_positions
+from spark.transfer.canonical import canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
 from tests.helpers.proportions import built, stout, striding, waving
 from tests.helpers.recorded import HIPS_UP, TRAVEL, answered, body, habits, performance
-from tests.helpers.stick import joint, scaled, stick_rig, without
+from tests.helpers.stick import joint, scaled, standing, stick_rig, without
 from tests.helpers.training import TINY, fresh
 
 ANKLES_UP = HABITS.index("ankles_up")
@@ -208,6 +208,24 @@ def test_a_checkpoint_says_what_was_learned(known: RecordedPairs, tmp_path: Path
     assert "unlike the characters of the training's recorded pairs" in far.notes[-1]
     np.testing.assert_array_equal(far.hips, fit_legs(source, transfer(source, wide)).hips)
     assert np.abs(near.hips - fit_legs(source, transfer(source, body(2))).hips).max() > 1e-3
+
+
+@pytest.mark.parametrize("near", [1.0, 0.8, 0.0])
+def test_by_what_recorded_pairs_do_not_tell_a_body_is_on_its_own_soles(
+    known: RecordedPairs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, near: float
+) -> None:
+    path = tmp_path / "checkpoint.safetensors"
+    save_checkpoint(replace(fresh(TINY), recorded=learn_recorded(known).tensors()), path)
+    retargeter = NetworkRetargeter(read_weights(path))
+    monkeypatch.setattr(KnownBodies, "nearness", lambda *_: near)
+    source, rig = to_canonical(standing(body(1), 40), body(1)), built(foot=1.2)
+    plain, told = transfer(source, rig), RecordedWeights(read_weights(path)).told
+    doubt = told.doubt(tokens_of(source.rig), tokens_of(rig))
+    recorded = as_recorded(told, source, plain, near**2, doubt=doubt).floor_z
+    own = 0.01 * rig.hip_height
+    expected = near**2 * recorded + (1.0 - near**2) * own
+    assert retargeter.fit_legs(source, plain).floor_z == pytest.approx(expected)
+    assert abs(recorded - own) > 1e-3
 
 
 def test_what_an_older_version_learned_is_refused(tmp_path: Path) -> None:
