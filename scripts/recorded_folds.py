@@ -30,6 +30,7 @@ from spark.training.recorded_ridge import Ridge, fit_ridge
 from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.own_soles import on_own_soles
 from spark.transfer.refine import refined
 
 FOLDS, SEED = 6, 0
@@ -97,7 +98,8 @@ def recorded_method(learned: Recorded, habits: HabitsOf) -> Method:
         share = learned.known.nearness(bodies[0]) * learned.known.nearness(bodies[1])
         doubt = None if isinstance(habits, Ridge) else learned.told.doubt(*bodies)
         moved = transfer(source, rig)
-        return as_recorded(habits, source, moved, share, bodies=bodies, doubt=doubt)
+        fitted = as_recorded(habits, source, moved, share, bodies=bodies, doubt=doubt)
+        return on_own_soles(source, fitted)
 
     return method
 

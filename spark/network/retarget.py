@@ -103,10 +103,10 @@ class NetworkRetargeter:
         moved: CanonicalMotion,
         recording: CanonicalMotion | None = None,
     ) -> CanonicalMotion:
-        """`moved`, the transfer of `source`, with its legs fitted: by the two bodies' proportions,
-        on its own soles (`spark.transfer.own_soles`: `recording` is a motion of the target's own),
-        and where the network learned from recorded pairs, and met bodies like these two, as
-        these have it (`spark.network.recorded`)."""
+        """`moved`, the transfer of `source`, with its legs fitted by the two bodies' proportions,
+        and where the network learned from recorded pairs, and met bodies like these two, as these
+        have it (`spark.network.recorded`); on its own soles (`spark.transfer.own_soles`:
+        `recording` is a motion of the target's own)."""
         if self.recorded is None:
             return fit_body(source, moved, recording)
         bodies = tokens_of(source.rig), tokens_of(moved.rig)
@@ -118,7 +118,7 @@ class NetworkRetargeter:
         told = self.recorded.told
         doubt = told.doubt(*bodies)
         fitted = as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
-        return on_own_soles(source, fitted, recording, 1.0 - share)
+        return on_own_soles(source, fitted, recording)
 
     def _blend_windows(
         self,

@@ -25,21 +25,18 @@ def fit_body(
 
 
 def on_own_soles(
-    source: CanonicalMotion,
-    moved: CanonicalMotion,
-    recording: CanonicalMotion | None = None,
-    share: float = 1.0,
+    source: CanonicalMotion, moved: CanonicalMotion, recording: CanonicalMotion | None = None
 ) -> CanonicalMotion:
-    """`moved`, a transfer of `source`, so high over z = 0 as its own soles are, or by a `share` of
-    the way: as high as in `recording`, a motion of its own, if that stands on z = 0, else as high
-    as usual. Itself where the two bodies have the same feet, or the source tells nothing."""
+    """`moved`, a transfer of `source`, so high over z = 0 as its own soles are: as high as in
+    `recording`, a motion of its own, if that stands on z = 0, else as high as usual. Itself where
+    the two bodies have the same feet, or the source tells nothing."""
     rig = moved.rig
-    if not share or same_feet(source.rig, rig) or not _steady_on_zero(source):
+    if same_feet(source.rig, rig) or not _steady_on_zero(source):
         return moved
     own = USUAL * rig.hip_height
     if recording is not None and on_zero(rig, recording.floor_z):
         own = float(np.clip(recording.floor_z, 0.0, THICKEST * rig.hip_height))
-    up = share * (own - moved.floor_z)
+    up = own - moved.floor_z
     return replace(moved, hips=moved.hips + np.array([0.0, 0.0, up]), floor_z=moved.floor_z + up)
 
 

@@ -9,7 +9,7 @@ from spark.rig.rig import Rig
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.leg_fit import fit_legs
-from spark.transfer.own_soles import fit_body, on_own_soles
+from spark.transfer.own_soles import fit_body
 from spark.transfer.refine import refined
 from spark.transfer.soles import lowest_soles
 from tests.helpers.proportions import built
@@ -77,13 +77,3 @@ def test_a_source_that_stands_on_two_heights_is_left_alone(climb: float) -> None
     source = replace(low, hips=hips, floor_z=low.floor_z + min(climb, 0.0))
     moved = transfer(source, OTHER_FEET[0])
     assert_same(fit_body(source, moved), fit_legs(source, moved))
-
-
-def test_a_share_goes_part_of_the_way() -> None:
-    source = stood(stick_rig())
-    legs = fit_legs(source, transfer(source, OTHER_FEET[0]))
-    whole, half = (on_own_soles(source, legs, share=share) for share in (1.0, 0.5))
-    np.testing.assert_allclose(half.hips, (legs.hips + whole.hips) / 2)
-    assert half.floor_z == pytest.approx((legs.floor_z + whole.floor_z) / 2)
-    assert whole.floor_z < legs.floor_z - 0.01
-    assert_same(on_own_soles(source, legs, share=0.0), legs)
