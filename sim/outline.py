@@ -77,12 +77,19 @@ def outline(
     return np.zeros((0, 3)), 0.0
 
 
+def all_around(
+    model: mujoco.MjModel, geom: int, looks: Float[np.ndarray, "D 3"], ring: int
+) -> Float[np.ndarray, "P 3"]:
+    """The points of `outline` [m], and where it has a radius, those on the balls around them: what
+    is round is looked at from `looks`."""
+    points, radius = outline(model, geom, ellipsoid=looks, mesh=looks, ring=ring)
+    return (points[:, None] + radius * looks).reshape(-1, 3) if radius else points
+
+
 def surface(model: mujoco.MjModel, geom: int, spacing: float) -> Float[np.ndarray, "P 3"]:
     """Points [m] all over a geom's convex hull, at most about `spacing` [m] from each other; of a
     round one to within a millimetre or two. A plane and a height field have none."""
-    points, radius = outline(model, geom, ellipsoid=_LOOKS, mesh=_LOOKS, ring=_RING)
-    if radius:
-        points = (points[:, None] + radius * _LOOKS).reshape(-1, 3)
+    points = all_around(model, geom, _LOOKS, _RING)
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):  # it is flat, or has no points

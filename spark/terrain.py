@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from spark.summary import brief
 
@@ -58,6 +56,9 @@ class Terrain:
 
     @cached_property
     def _parts(self) -> tuple[Int[np.ndarray, "F"], Bool[np.ndarray, "K"]]:
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components  # slow, and few motions state ground
+
         size = max(float(np.ptp(self.vertices, axis=0).max(initial=0.0)), 1e-9)
         grid = np.round(self.vertices / (_SAME * size))
         same = np.unique(grid, axis=0, return_inverse=True)[1].reshape(-1)[self.faces]

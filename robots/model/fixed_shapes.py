@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from robots.model.compiling import compiled_or_cached
 from robots.model.mjcf import parse_model
-from sim.outline import fibonacci_sphere, outline, solid
+from sim.outline import all_around, fibonacci_sphere, solid
 from spark.errors import FileFormatError
 from spark.io.terrain_file import checked
 from spark.terrain import Terrain
@@ -60,9 +60,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
         return vertices.astype(np.float64), faces.astype(np.int64)
     if kind == _HFIELD:
         return _height_field(model, int(model.geom_dataid[geom]))
-    points, radius = outline(model, geom, ellipsoid=_LOOKS, mesh=_LOOKS, ring=_RING)
-    if radius:
-        points = (points[:, None] + radius * _LOOKS).reshape(-1, 3)
+    points = all_around(model, geom, _LOOKS, _RING)
     hull = ConvexHull(points)
     a, b, c = points[hull.simplices].swapaxes(0, 1)
     inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
 from robots.model.mjcf import Mjcf
-from sim.outline import outline, solid
+from sim.outline import all_around, solid
 from spark.rotation import quat_between
 
 _NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole
@@ -35,9 +35,7 @@ def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
 
 def surface_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Float[np.ndarray, "P 3"]:
     """Points on one shape, where `data` places it; none for what has no surface of its own."""
-    points, radius = outline(model, geom, ellipsoid=DIRECTIONS, mesh=DIRECTIONS, ring=_RING)
-    if radius:
-        points = (points[:, None] + radius * DIRECTIONS).reshape(-1, 3)
+    points = all_around(model, geom, DIRECTIONS, _RING)
     rotation = data.geom_xmat[geom].reshape(3, 3)
     return points @ rotation.T + data.geom_xpos[geom]
 

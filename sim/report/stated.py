@@ -34,11 +34,10 @@ def stated_ground(
     there: as high as they do in the median, as a recording's floor is where its feet are."""
     own = course.subject.terrain
     theirs = None if source is None else source.subject.terrain
-    if own is None and theirs is None:
-        return None
-    if own is None and theirs is not None:
+    if own is None:
+        if theirs is None:
+            return None
         own = theirs.placed(scale, np.zeros(3))
-    assert own is not None
     ground = replace(level_ground(0.0), terrain=own)
     notes = (
         f"the ground is stated, up to {100 * own.vertices[:, 2].max():.0f} cm high: all heights "
@@ -50,24 +49,15 @@ def stated_ground(
         return Stated(ground, replace(level_ground(0.0), terrain=theirs), notes)
     under = _under_source(source, own.placed(1.0 / scale, np.zeros(3)))
     if under is None:
-        return Stated(
-            ground,
-            None,
-            (
-                *notes,
-                "the source is not on it, scaled to its size: it is "
-                "judged on what its own feet tell",
-            ),
+        where = (
+            "the source is not on it, scaled to its size: it is judged on what its own feet tell"
         )
-    return Stated(
-        ground,
-        under,
-        (
-            *notes,
-            f"the source is on it scaled by {1 / scale:.3g}, over a "
-            f"floor at z = {under.floor_z:.2f} m, where its feet stand in the median",
-        ),
-    )
+    else:
+        where = (
+            f"the source is on it scaled by {1 / scale:.3g}, over a floor at "
+            f"z = {under.floor_z:.2f} m, where its feet stand in the median"
+        )
+    return Stated(ground, under, (*notes, where))
 
 
 def _under_source(source: Course, terrain: Terrain) -> Ground | None:
@@ -84,8 +74,7 @@ def _under_source(source: Course, terrain: Terrain) -> Ground | None:
         held = footholds(placed, floor_z, paths, lowest, still, size)
         sunk = placed.way_up(paths.mean(axis=2).reshape(-1, 3)).reshape(still.shape)
         stands = held.stands & (sunk < _SUNK * size)
-        below = held.heights + np.minimum(held.relief.min(axis=2), 0.0)
-        over = float(np.median((lowest - below)[stands])) if stands.any() else 0.0
+        over = float(np.median((lowest - held.lowest)[stands])) if stands.any() else 0.0
         found.append((int(stands.sum()), floor_z + over))
     most, floor_z = max(found, key=lambda each: each[0])
     if most < _FITS * still.sum() or not still.any():

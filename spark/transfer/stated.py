@@ -39,6 +39,11 @@ class Footholds(NamedTuple):
     heights: Float[np.ndarray, "T S"]
     relief: Float[np.ndarray, "T S 2"]
 
+    @property
+    def lowest(self) -> Float[np.ndarray, "T S"]:
+        """The height [m, world] of what is below the lowest point of a foot that lies on it."""
+        return self.heights + np.minimum(self.relief.min(axis=2), 0.0)
+
 
 def footholds(
     terrain: Terrain,
@@ -94,8 +99,7 @@ def on_terrain(source: CanonicalMotion, terrain: Terrain) -> CanonicalMotion:
         )
     if not held.stands.any():
         return replace(source, terrain=terrain, floor_z=floor_z, notes=(*source.notes, *notes))
-    below = held.heights + np.minimum(held.relief.min(axis=2), 0.0)
-    over = np.where(held.stands, lowest - below, np.nan)
+    over = np.where(held.stands, lowest - held.lowest, np.nan)
     off = float(np.nanmedian(over))
     if abs(off) > _OFF * scale:
         side = "above" if off > 0 else "below"
@@ -132,7 +136,7 @@ def _floor(
 ) -> float:
     """The height of the floor [m, world]; feet that stand `beside` the terrain are on it."""
     base = float(terrain.vertices[:, 2].min())
-    on = (held.heights + np.minimum(held.relief.min(axis=2), 0.0))[held.stands]
+    on = held.lowest[held.stands]
     if not len(on):
         seen = floor_z
     else:
